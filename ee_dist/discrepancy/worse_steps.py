@@ -23,6 +23,10 @@ MUCH, MOST_OF_IT = 1.5, 0.5
 """Times its error by which a channel got much worse, and its share of all that channels got worse by, to be named."""
 
 
+FARTHER = 1.1
+"""Times the least error of a step from which it is told that the model ends farther off."""
+
+
 @dataclass(frozen=True)
 class WorseStep:
     """The step ``number`` of the ladder, which took the error on these trials from ``before`` to ``after`` (not ``overall``: made
@@ -55,6 +59,13 @@ def worse_steps(problem: Problem, steps: Sequence[StepApart]) -> list[WorseStep]
     return out
 
 
+def nearest_step(steps: Sequence[StepApart]) -> int | None:
+    """The number of the step after which least was left of these trials, where clearly more is left in the end: several steps,
+    none of which made them worse by more than chance, may do so together. None where the first or the last is the nearest."""
+    k = int(np.argmin([s.error for s in steps]))
+    return k if 0 < k < len(steps) - 1 and steps[-1].error > FARTHER * steps[k].error else None
+
+
 def _much_worse(a: StepApart, b: StepApart, last: StepApart) -> int | None:
     """The channel at which most of what got worse is, and that got much worse for good; None where no single one did."""
     if not np.isfinite(b.error):
@@ -78,7 +89,15 @@ def worse_step_lines(word: LastWord | None, ladder: Sequence[Rung]) -> list[str]
     if word is None:
         return []
     found = worse_steps(word.problem, word.steps)
-    return [_text(word.problem, step, ladder[step.number]) for step in found]
+    lines = [_text(word.problem, step, ladder[step.number]) for step in found]
+    nearest = nearest_step(word.steps) if word.steps else None
+    if nearest is not None and not any(s.overall and s.number > nearest for s in found):
+        least, last = (word.problem.told(word.steps[k].error) for k in (nearest, -1))
+        lines.append(
+            f"On {TRIALS_APART} least was left after step {nearest} of the ladder, {least}, and {last} after its last: what "
+            "came in between may suit the fitted motions alone."
+        )
+    return lines
 
 
 def _text(problem: Problem, step: WorseStep, rung: Rung) -> str:

@@ -140,3 +140,23 @@ def test_of_two_laws_that_data_do_not_tell_apart_both_go_first_where_they_take_o
         )
     ]
     assert len(ranked(found)[0].proposal.parts) == first
+
+
+@pytest.mark.parametrize(("alone", "first"), [(17.0, 2), (15.0, 1)])
+def test_one_number_goes_before_two_that_it_is_tied_with_unless_they_take_off_twice_as_much(
+    alone: float, first: int
+) -> None:
+    """Of few motions an interval holds nearly anything: a pendulum that rubs was told to be heavier."""
+    problem = Linear((), motions=4)
+    unit = np.sign(problem.data)
+    one, *two = (candidate(ROBOT, e, j) for e, j in (
+        ("motor_weak", "knee_front_left"), ("coulomb_friction", "knee_front_left"), ("coulomb_friction", "hip_rear_left")
+    ))  # fmt: skip
+    uneven = np.where(problem.trial_of == 0, 20.0, 9.0) * unit
+    models = [Proposal((one,)), Proposal(tuple(two))]
+    found = [
+        judge(problem, 20.0 * unit, held_out(problem, r, True, p.parts), p, Model(p.parts), 10)
+        for p, r in zip(models, (alone * unit, uneven), strict=True)
+    ]
+    order = ranked(found)
+    assert len(order[0].proposal.parts) == first and order[0].tied_with == [order[1].name]

@@ -117,7 +117,7 @@ def test_a_guess_goes_before_as_many_numbers_that_it_is_tied_with(
     def judged(name: str, size: int, guess: bool, left: float) -> SimpleNamespace:
         proposal = SimpleNamespace(parts=(), size=size, guess=guess)
         return SimpleNamespace(
-            name=name, proposal=proposal, vague=False, earned=True, stands=True, held=np.array([left])
+            name=name, proposal=proposal, vague=False, earned=True, stands=True, held=np.array([left]), gain=10.0 - left
         )
 
     found = [judged("most", 12, False, 1.0), judged("each", 6, False, 1.2), judged("guess", size, True, 1.3)]

@@ -17,7 +17,7 @@ from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.last_word import TRIALS_APART, last_word
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.steps_apart import step_apart
-from ee_dist.discrepancy.worse_steps import worse_steps
+from ee_dist.discrepancy.worse_steps import nearest_step, worse_step_lines, worse_steps
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.effects.model_file import read_model
 from ee_dist.trials.log import Array
@@ -131,3 +131,28 @@ def test_what_a_later_step_brings_back_is_not_told_and_one_joint_is_although_all
     loud = replace(first, off=np.array([1.0, 3.0]), error=2.2, energy=np.tile([[20.0, 180.0]], (20, 1)))
     (step,) = worse_steps(apart, [quiet, loud])
     assert not step.overall and step.channel == "b" and step.at == (1.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("errors", "nearest"), [((5, 2, 2.1, 2.3), 1), ((5, 2, 2.1, 2.15), None), ((5, 6, 7), None), ((5, 4, 3), None)]
+)
+def test_steps_that_make_it_worse_together_are_told_by_the_one_after_which_least_was_left(
+    errors: tuple[float, ...], nearest: int | None
+) -> None:
+    """None of them by more than what one segment differs from the next by."""
+    problem, apart = Linear(HIDDEN, motions=4), Linear(HIDDEN, seed=7)
+    found, word = stepped(problem, apart)
+    rng = np.random.default_rng(2)
+    energies = [e**2 * rng.exponential(size=(20, 2)) for e in errors]
+    steps = tuple(
+        replace(word.steps[0], error=e, energy=en, off=np.ones(2)) for e, en in zip(errors, energies, strict=True)
+    )
+    assert nearest_step(steps) == nearest
+    ladder = [*found.ladder, *found.ladder][: len(steps)]
+    lines = worse_step_lines(replace(word, steps=steps), ladder)
+    told = [line for line in lines if "least was left after step" in line]
+    assert len(told) == (
+        nearest is not None and not any(s.overall and s.number > nearest for s in worse_steps(apart, steps))
+    )
+    if told:
+        assert f"{apart.told(2)}, and {apart.told(2.3)} after its last" in told[0]

@@ -28,7 +28,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         found = SimpleNamespace(
             ladder=[start, rung], left=[], verdict=verdict, explained=share, parameters=[], terms=rung.added, stopped="so",
             noise_floor=1.0, floor_source="told", last=None, odd=[], worth=None, unsure=[], twins=[],
-            judged_on=rung.held_out, all_rows=None, at_limit=[],
+            judged_on=rung.held_out, all_rows=None, at_limit=[], no_farther=(),
         )  # fmt: skip
         account = improve_account(problem, found)  # type: ignore[arg-type]
         assert account.headline.endswith(said) or said in account.headline

@@ -237,7 +237,9 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
     if ordered:
         # Of explanations that data do not tell apart the one with the fewest numbers says the least that is not known.
         best = ordered[0]
-        same = [best, *(j for j in ordered[1:] if j.earned and j.name in best.tied_with)]
+        # Few motions tie nearly all: what takes off less than half as much is named, and does not go first for being short.
+        as_good = [j for j in ordered[1:] if j.gain >= HALF * best.gain]
+        same = [best, *(j for j in as_good if j.earned and j.name in best.tied_with)]
         # Of as many, a number that was only assumed is blamed before parts that somebody vouched for.
         first = min(same, key=_least_said)
         # What was only guessed at is asked for before as many numbers that are tied with it, be these tied with a better one too.
