@@ -42,6 +42,7 @@ class Following:
 
     def __init__(self, one: SimpleNamespace) -> None:
         self.__dict__.update(one.__dict__)
+        self.gain = self.explained
 
     @property
     def earned(self) -> bool:
