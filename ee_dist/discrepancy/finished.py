@@ -36,7 +36,7 @@ def finished(
     last: Examined | None,
     twins: list[Twin],
     tried: int,
-    no_farther: frozenset[str] = frozenset(),
+    no_farther: frozenset[str],
 ) -> Improvement:
     """The result of a search that climbed the ``ladder`` from the residual ``base`` (n,) and ``stopped`` with ``current``;
     ``last``: what was tried on top of it, ``tried``: of how many effects it chose; ``no_farther``:

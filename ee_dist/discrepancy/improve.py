@@ -110,9 +110,7 @@ def improve(
             judged = _asked(search, current, as_long(problem, c))
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
-        if (wider := with_more_room(search, current.parts, current.u)) is not None:
-            current = Current(wider.parts, wider.u)
-            climb(refitted(search, current, MORE_ROOM))
+        current = _roomier(search, current, climb) or current
         no_farther = guesses_at_end(current.parts, current.u)
     else:
         exchanges, spread, anew, refused, nor = 0, 0, 0, 0, ""
@@ -170,9 +168,8 @@ def improve(
                     climb(rung)
                     continue
                 # Beside all that came since, a guess may be farther off than it could go when it was put right.
-                if (wider := with_more_room(search, current.parts, current.u)) is not None:
-                    current = Current(wider.parts, wider.u)
-                    climb(refitted(search, current, MORE_ROOM))
+                if (wider := _roomier(search, current, climb)) is not None:
+                    current = wider
                     continue
                 no_farther = guesses_at_end(current.parts, current.u)
                 why_not = WORSE if worse else last.judged[0].why_not if last.judged else LUCK
@@ -215,6 +212,17 @@ def improve(
         )
     tried = 0 if wanted is not None else len(pool)
     return finished(search, current, ladder, as_it_is, stopped, last, twins, tried, no_farther)
+
+
+def _roomier(search: Search, current: Current, climb: Callable[[Rung], None]) -> Current | None:
+    """The model with more room for guesses that ended at an end of theirs, as a step of the ladder; None where that is not worth
+    one."""
+    wider = with_more_room(search, current.parts, current.u)
+    if wider is None:
+        return None
+    found = Current(wider.parts, wider.u)
+    climb(refitted(search, found, MORE_ROOM))
+    return found
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:

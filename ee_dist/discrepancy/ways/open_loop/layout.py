@@ -47,7 +47,7 @@ def lay_out(
         middle = _middles(robot, part, filled, block)
         time += [np.repeat(middle, s), np.repeat(_middles(robot, part, filled, window), 2 * s)]
         reading += [np.ones(blocks * s, dtype=bool), np.zeros(2 * windows * s, dtype=bool)]
-        least, left = weights.floors(k, soft, robot)
+        least, left = weights.floors(k, soft)
         floor += least
         known += left
         if isinstance(part.run.driver, Network):

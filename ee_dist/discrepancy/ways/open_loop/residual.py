@@ -28,7 +28,7 @@ def residual_of(
     grain = grain_of(measured, weights.rough(predicted), weights.tiny) / weights.grain_deviation[part]
     compared = np.array([x.kind not in weights.repeating for x in robot.sensors])
     texture = np.stack(
-        [grain * weights.smooth(robot), frozen(measured, predicted, weights.window) * compared * moving], axis=1
+        [grain * weights.smooth, frozen(measured, predicted, weights.window) * compared * moving], axis=1
     )
     return np.concatenate([soften(v[..., own], soft).ravel() for v in (shape, texture)])
 

@@ -45,7 +45,8 @@ class Weights:
     moves block means, ``known`` (2, S) mean squares that calibration left of both.
 
     ``undeclared`` (S,) is the variance of noise that no description declares; most sensors of the kinds in ``repeating``
-    repeat readings more often than the model's, and of those in ``rugged`` it is not compared how rough they are either.
+    repeat readings more often than the model's, and of those in ``rugged`` it is not compared how rough they are either:
+    ``smooth`` (S,) are the channels of which it is.
     """
 
     scale: Scale
@@ -58,6 +59,7 @@ class Weights:
     undeclared: Array
     repeating: frozenset[str]
     rugged: frozenset[str]
+    smooth: Mask
     own: tuple[Array, ...]
     """Places of the channels that were recorded in each part: nothing is compared of others."""
 
@@ -70,11 +72,7 @@ class Weights:
         """(windows, S) of a prediction, with the noise that no description declares."""
         return _rough(predicted, self.undeclared, self.tiny)
 
-    def smooth(self, robot: Robot) -> Mask:
-        """(S,) channels of which it is compared how rough they are."""
-        return np.array([x.kind not in self.rugged for x in robot.sensors])
-
-    def floors(self, part: int, soft: float, robot: Robot) -> tuple[list[Array], list[Array]]:
+    def floors(self, part: int, soft: float) -> tuple[list[Array], list[Array]]:
         """Mean squares of a part's values under a perfect model, and what of them is no noise: of means (blocks * S,), then of
         texture (windows * 2 * S,)."""
         # How far noise moves the log of roughness beside what is too small to count, as a share of what it does alone.
@@ -86,7 +84,7 @@ class Weights:
         share = (noise / self.block + self.begun[part]) / off + left
         rough = _ROUGH_FLOOR * texture / grain_off
         grain = _ROUGH_FLOOR * noisy * pure / grain_off + rough
-        grain, rough = grain * self.smooth(robot), rough * self.smooth(robot)
+        grain, rough = grain * self.smooth, rough * self.smooth
         share, left, grain, rough = (values[:, self.own[part]] for values in (share, left, grain, rough))
         floor = [share.ravel() * _SOFT_FLOOR[soft], np.stack([grain, np.zeros_like(grain)], axis=1).ravel()]
         return floor, [left.ravel() * _SOFT_FLOOR[soft], np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
@@ -124,16 +122,33 @@ def weigh(
             grain = np.mean([np.log(_rough(d, undeclared, tiny) / usual) ** 2 for d in others], axis=0)
         deviation.append(np.sqrt(noise + _held_up(spread)))
         grain_deviation.append(np.sqrt(_by_luck(window) + known[k][1] + _held_up(grain)))
-    rugged: frozenset[str] = frozenset()
-    if bare:
-        each = [(d, p, tells, own) for d, p, tells, own in zip(data, first, moving, recorded, strict=True) if p.finite]
-        grains = [grain_of(d, _rough(p, undeclared, tiny), tiny) ** 2 / _by_luck(window) for d, p, _, _ in each]
-        again = [(frozen(d, p, window) * tells) ** 2 for d, p, tells, _ in each]
-        rugged = most_odd(
-            robot, [(g + a, own) for g, a, (_, _, _, own) in zip(grains, again, each, strict=True) if len(g)]
-        )
-    settled = tuple(deviation), tuple(grain_deviation), begun, tuple(known), undeclared, repeats | rugged, rugged
+    compared = list(zip(data, first, moving, recorded, strict=True)) if bare else []
+    rugged = _rugged(robot, compared, undeclared, tiny, window)
+    smooth = np.array([x.kind not in rugged for x in robot.sensors])
+    settled = (
+        tuple(deviation),
+        tuple(grain_deviation),
+        begun,
+        tuple(known),
+        undeclared,
+        repeats | rugged,
+        rugged,
+        smooth,
+    )
     return Weights(scale, block, window, *settled, tuple(map(np.flatnonzero, recorded)))
+
+
+def _rugged(
+    robot: Robot, trials: Sequence[tuple[Digest, Digest, Mask, Mask]], undeclared: Array, tiny: Array, window: int
+) -> frozenset[str]:
+    """Kinds of sensors most of which are rougher than the model's, or repeat readings otherwise, from (measured, predicted, where
+    repeats tell, which channels were recorded) of each trial."""
+    squares = []
+    for measured, predicted, tells, recorded in trials:
+        if predicted.finite and len(predicted.rough):
+            grain = grain_of(measured, _rough(predicted, undeclared, tiny), tiny) ** 2 / _by_luck(window)
+            squares.append((grain + (frozen(measured, predicted, window) * tells) ** 2, recorded))
+    return most_odd(robot, squares)
 
 
 def _tiny(scale: Scale) -> Array:
